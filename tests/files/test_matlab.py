@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from scipy.io import savemat
+from scipy.sparse import csc_array
 
 from mrhubo import UserError
 from mrhubo.files import matlab
@@ -43,13 +44,23 @@ def test_what_is_refused_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path
     path.write_bytes(path.read_bytes()[:300])
     with pytest.raises(UserError, match=r"take\.mat: is a MATLAB file that is damaged"):
         read_tree(path)
-    monkeypatch.setattr(matlab, "_MAX_NUMBERS", 20)
-    savemat(path, _VALUES)
-    with pytest.raises(UserError, match="'places' has more than 20 numbers; cut it"):
+    savemat(path, {"structure": {"zeros": np.zeros(10**6)}}, do_compression=True)  # a thousandth of it
+    monkeypatch.setattr(matlab, "_MAX_BYTES", 10**6)
+    with pytest.raises(UserError, match=r"take\.mat: has more than 1,000,000 bytes when it is unpacked; cut it"):
         read_tree(path)
     monkeypatch.setattr(matlab, "_MAX_BYTES", 200)
     with pytest.raises(UserError, match="at most 200 bytes are read"):
         read_tree(path)
+
+
+def test_what_is_no_number_and_no_text_is_nothing(tmp_path: Path) -> None:
+    """Sparse and complex numbers, and lists of more than one kind."""
+    path = tmp_path / "take.mat"
+    cells = np.array([1.5, "x", np.array([1.0, 2.0])], dtype=object)
+    savemat(path, {"sparse": csc_array(np.eye(3)), "complex": np.ones(3) * 1j, "cells": cells, "is": np.array([True])})
+    tree = read_tree(path)
+    assert tree["sparse"].is_none and tree["complex"].is_none
+    assert [child.text() or child.shape() for child in tree["cells"]] == [(), "x", (2,)]
 
 
 @given(steps=accidents)

@@ -45,8 +45,8 @@ _NUMBERS = ("frame_id", "frame", "frame_idx", "frame_index", "frame_number")
 _IDS = ("track_id", "body_id", "person_id", "id")
 _PICTURE = "image_id"
 """What lists of detections, as COCO has them, call the frame in which somebody was seen."""
-_FEWEST, _MOST_VALUES = 2, 10**7
-"""Frames of a list in a container other than JSON, at least; and values in that, at most."""
+_FEWEST, _MOST_VALUES, _DEEPEST = 2, 10**7, 10
+"""Frames of a list in a container other than JSON, at least; values in that, and lists in lists, at most."""
 _DIGIT = re.compile(r"[0-9]")
 
 
@@ -107,7 +107,7 @@ def points_of_frames(tree: Tree, options: ReadOptions) -> Keypoints | None:
     if frames is None or len(frames) < _FEWEST:
         return None
     try:
-        value = _plain(tree, [_MOST_VALUES])
+        value = _plain(tree, [_MOST_VALUES], _DEEPEST)
         found = points_of_json(tree.path, value, options)
     except NoMotion:
         return None
@@ -118,18 +118,25 @@ def points_of_frames(tree: Tree, options: ReadOptions) -> Keypoints | None:
     return found if by_names(found.names or ()).keys() >= set(NEEDED) else None
 
 
-def _plain(node: Tree, left: list[int]) -> Any:
-    """What a node holds, as JSON would have it; `left`: how many values more may be in it."""
-    left[0] -= 1
+def _plain(node: Tree, left: list[int], deepest: int) -> Any:
+    """What a node holds, as JSON would have it.
+
+    Args:
+        node: of any container.
+        left: how many values more may be in it.
+        deepest: dictionaries and lists in each other, at most.
+
+    Raises:
+        NoMotion: there is too much in it.
+    """
+    shape = None if node.is_mapping else node.shape()
+    left[0] -= 1 + math.prod(shape or (0,))
+    if left[0] < 0 or deepest < 0:
+        raise NoMotion(f"{node.path}: has more than {_MOST_VALUES:,} values, or lists in lists")
     if node.is_mapping:
-        return {name: _plain(child, left) for name, child in node.items()}
-    shape = node.shape()
+        return {name: _plain(child, left, deepest - 1) for name, child in node.items()}
     if shape is None and node.is_list:
-        return [_plain(child, left) for child in node]
-    if shape is not None:
-        left[0] -= math.prod(shape)
-    if left[0] < 0:
-        raise NoMotion(f"{node.path}: has more than {_MOST_VALUES:,} values")
+        return [_plain(child, left, deepest - 1) for child in node]
     return node.text() if shape is None else node.array().tolist()
 
 

@@ -15,13 +15,14 @@ from mrhubo.robot_motion.clock import find_rate as find_even_rate
 
 RATE_KEYS = (
     "mocap_frame_rate", "mocap_framerate", "frame_rate", "framerate", "frameRate", "fps", "FPS", "video_fps",
-    "motion_fps", "mocap_fps", "sample_rate", "sampling_rate", "sampleRate", "samplingRate", "sampling_frequency",
-    "frames_per_second", "hz", "Hz",
+    "motion_fps", "mocap_fps", "frames_per_second",
 )  # fmt: skip
 """What files call it; the first two are AMASS's."""
 TIME_KEYS = ("timestamps", "timestamps_s", "timestamps_ms", "timestamps_us", "timestamps_ns", "timestamp", "times",
              "time", "frame_times", "frame_timestamps")  # fmt: skip
 """What files call the times of their frames."""
+_SAMPLE_KEYS = ("sample_rate", "sampling_rate", "sampleRate", "samplingRate", "sampling_frequency", "hz", "Hz")
+"""What files may call it, if it is one of frames and not of a sound beside them."""
 _STEP_KEYS = ("dt", "frame_time", "frametime", "frameTime", "time_step", "timestep")
 """What files call the time from a frame to the next [s]."""
 _UNITS = (1.0, 1e-3, 1e-6, 1e-9)
@@ -73,6 +74,10 @@ def rate_in(node: Tree, notes: list[str]) -> tuple[str, float] | None:
             if number is not None:
                 return key, number
             open_ones.append(f"'{key}' tells no frame rate{_in_words(node[key])}")
+    for key in _SAMPLE_KEYS:
+        number = number_told(node[key]) if key in keys else None
+        if number is not None and RATES[0] <= number <= RATES[1]:
+            return key, number
     for key in TIME_KEYS:
         number = rate_of_times(node[key]) if key in keys else None
         if number is not None:

@@ -135,3 +135,25 @@ def test_numbers_of_frames_and_uneven_times_tell_none(times: Any, tmp_path: Path
         read_motion(tmp_path / "a")
     write("pickle", tmp_path / "a", timestamps=times, video_fps=25)
     assert read_motion(tmp_path / "a").frame_rate == 25
+
+
+@pytest.mark.parametrize(
+    ("told", "rate"),
+    [
+        ({"sample_rate": 60}, 60),
+        ({"dt": 0.02}, 50),
+        ({"sample_rate": 44_100, "dt": 0.02}, 50),  # a sound's
+        ({"sample_rate": 100, "fps": 25}, 25),
+        ({"dt": 33, "sampling_rate": 16_000}, None),
+    ],
+)
+def test_other_words_for_a_rate_are_believed_if_they_may_be_one(
+    told: dict[str, float], rate: float | None, tmp_path: Path
+) -> None:
+    path = tmp_path / "a.npz"
+    write("npz", path, **told)
+    if rate is None:
+        with pytest.raises(UserError, match="--rate"):
+            read_motion(path)
+    else:
+        assert read_motion(path).frame_rate == rate

@@ -84,7 +84,8 @@ def _read(path: Path, data: mmap.mmap) -> C3d:
     scale = float(told.number("POINT", "SCALE", float(scale)))
     start = int(told.number("POINT", "DATA_START", int(header[8]))) or int(header[8])
     rate = _rate(told.number("POINT", "RATE", header_rate), header_rate)
-    segments = _read_segments(path, data, told, last - first + 1, rate)
+    begin = (start - 1) * BLOCK
+    segments = _read_segments(path, data, told, last - first + 1, rate, begin if points or analog else len(data))
     if not points:
         if segments is None:
             raise UserError(f"{path}: is a C3D file without points; export it with the markers")
@@ -93,7 +94,6 @@ def _read(path: Path, data: mmap.mmap) -> C3d:
         raise UserError(f"{path}: is a C3D file whose points' scale is {scale}; is it damaged?")
     width = 4 if scale < 0 else 2
     stride = width * (4 * points + analog)
-    begin = (start - 1) * BLOCK
     there = max(0, len(data) - begin) // stride if begin >= 0 else 0
     frames = _frames([last - first + 1, told.long_range() or 0, int(told.number("POINT", "FRAMES", 0))], there)
     count = min(frames, there)
@@ -111,7 +111,9 @@ def _read(path: Path, data: mmap.mmap) -> C3d:
     return C3d(point_TK3, told.labels("POINT", points), rate, frames, segments)
 
 
-def _read_segments(path: Path, data: mmap.mmap, told: Parameters, frames: int, rate: float | None) -> Segments | None:
+def _read_segments(
+    path: Path, data: mmap.mmap, told: Parameters, frames: int, rate: float | None, points_at: int
+) -> Segments | None:
     """The segments, if there are any.
 
     Args:
@@ -120,13 +122,14 @@ def _read_segments(path: Path, data: mmap.mmap, told: Parameters, frames: int, r
         told: its parameters.
         frames: how many the header tells.
         rate: that of points.
+        points_at: where their frames begin.
     """
     count, start = (int(told.number("ROTATION", name, 0)) for name in ("USED", "DATA_START"))
     begin, stride = (start - 1) * BLOCK, 4 * _OF_SEGMENT * count
     if count < 1 or begin < 0:
         return None
     ratio = max(1, int(told.number("ROTATION", "RATIO", 1)))
-    there = max(0, len(data) - begin) // stride
+    there = max(0, (points_at if points_at > begin else len(data)) - begin) // stride
     counts = [int(told.number("ROTATION", "FRAMES", 0)), ratio * frames, frames, told.long_range() or 0]
     length = min(_frames(counts, there), there)
     if length < 1:

@@ -84,6 +84,24 @@ def test_matrices_names_and_rate_come_back(processor: int, ratio: int, frames_to
     np.testing.assert_allclose(found.place_TS3, matrix_TS44[..., :3, 3], atol=1e-3)
 
 
+def test_frames_of_points_are_none_of_segments(tmp_path: Path) -> None:
+    """Of a file without the count of those, whose ratio would make more frames of what follows."""
+    path, segmented = tmp_path / "pose.c3d", theia()
+    data = bytearray(c3d(*marked(), Manner(analog=300), replace(segmented, frames_told=False)))
+    starts = [data.index(b"DATA_START") + len("DATA_START") + 4]
+    header, rotation = int.from_bytes(data[16:18], "little"), int.from_bytes(data[starts[0] : starts[0] + 2], "little")
+    points, turns = data[512 * (header - 1) : 512 * (rotation - 1)], data[512 * (rotation - 1) :]
+    swapped = data[: 512 * (header - 1)] + turns + points
+    ratio = swapped.index(b"RATIO") + len("RATIO") + 4
+    swapped[ratio : ratio + 2] = (2).to_bytes(2, "little")
+    swapped[starts[0] : starts[0] + 2] = data[16:18]
+    swapped[16:18] = (header + len(turns) // 512).to_bytes(2, "little")
+    path.write_bytes(bytes(swapped))
+    found = read_c3d_file(path)
+    assert found.segments is not None and len(found.segments.turn_TS33) == 60 and len(found.point_TK3) == 60
+    np.testing.assert_allclose(found.point_TK3, marked()[0], atol=1e-3)
+
+
 @pytest.mark.parametrize(
     ("unit", "world_33", "said"),
     [(1000.0, _Z_UP, "millimetres, z up"), (1.0, np.eye(3), "metres, y up")],
