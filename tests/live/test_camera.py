@@ -98,7 +98,10 @@ def test_a_camera_that_is_unplugged_stops_the_robot_and_ends_the_session(cv2: An
         run_session(session)
     assert poses and session.last is not None and session.last.state == "ended"
     assert not session.last.velocity_N.any(), "it has braked"
-    assert not [thread for thread in threading.enumerate() if thread.name.startswith("camera")]
+    until = time.monotonic() + 60.0  # a look at a picture that has begun is ended, however busy the machine is
+    while [thread for thread in threading.enumerate() if thread.name.startswith("camera")]:
+        assert time.monotonic() < until, "a thread goes on"
+        time.sleep(0.01)
 
 
 def test_the_newest_picture_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -175,7 +178,10 @@ def test_a_film_that_shows_one_picture_for_long_ends_at_once(tmp_path: Path, fig
     path = write_video(tmp_path / "film.mkv", [figure, figure, figure], [0, 40, 60_000])
     session, _ = followed(CameraSource(film=path, model="lite"))
     run_session(session, 0.5)
-    assert not [thread for thread in threading.enumerate() if thread.name.startswith("camera")]
+    until = time.monotonic() + 60.0  # a look at a picture that has begun is ended, however busy the machine is
+    while [thread for thread in threading.enumerate() if thread.name.startswith("camera")]:
+        assert time.monotonic() < until, "a thread goes on"
+        time.sleep(0.01)
 
 
 def test_a_damaged_film_ends_the_session_with_a_sentence(film: Path, tmp_path: Path) -> None:
