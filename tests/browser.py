@@ -21,7 +21,7 @@ import numpy as np
 import pytest
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
-_PATIENCE = 30.0
+_PATIENCE = 120.0
 
 
 def find_browser() -> str:
@@ -79,7 +79,7 @@ class Browser:
         port = port_file.read_text().split("\n")[0]
         from websockets.sync.client import connect
 
-        with urlopen(f"http://127.0.0.1:{port}/json/list", timeout=10) as answer:
+        with urlopen(f"http://127.0.0.1:{port}/json/list", timeout=60) as answer:
             target = next(one for one in json.load(answer) if one["type"] == "page")
         self._socket = connect(target["webSocketDebuggerUrl"], max_size=2**26)
         for domain in ("Page", "Runtime", "Log"):
@@ -94,7 +94,7 @@ class Browser:
         self._socket.close()
         self._process.terminate()
         try:
-            self._process.wait(10)
+            self._process.wait(30)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()

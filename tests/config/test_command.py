@@ -208,7 +208,7 @@ def test_a_signal_while_llvm_tells_what_it_has_compiled_is_not_lost(number: sign
     assert process.stdout is not None and process.stdout.readline() == "go\n"
     process.send_signal(number)
     try:
-        _, err = process.communicate(timeout=30)
+        _, err = process.communicate(timeout=120)
     finally:
         process.kill()
     word = "interrupted" if number == signal.SIGINT else "terminated"
@@ -231,6 +231,6 @@ def test_a_library_that_catches_everything_while_it_is_imported_loses_no_signal(
     assert process.stdout is not None and process.stdout.readline() == "go\n"
     for _ in range(2):  # who is impatient presses twice
         process.send_signal(number)
-    _, err = process.communicate(timeout=30)
+    _, err = process.communicate(timeout=120)
     word = "interrupted" if number == signal.SIGINT else "terminated"
     assert (process.returncode, err) == (128 + number, f"{word}; the same command resumes\n")

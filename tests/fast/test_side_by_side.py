@@ -33,7 +33,7 @@ def test_results_are_in_the_order_of_the_items() -> None:
 
 @pytest.mark.skipif(available_cores() < 2, reason="one core: nothing goes side by side")
 def test_it_goes_in_threads_of_which_the_callers_is_one() -> None:
-    both = threading.Barrier(2, timeout=30)
+    both = threading.Barrier(2, timeout=120)
 
     def work(_: int) -> str:
         both.wait()  # is passed by two threads at a time alone

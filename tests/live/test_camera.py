@@ -83,7 +83,7 @@ def test_a_film_is_followed_as_if_a_camera_saw_it(film: Path, figure: np.ndarray
         session, poses = followed(source)
         begun = time.monotonic()
         run_session(session)
-        assert 1.3 < time.monotonic() - begun < 30.0, "a film is played at its own pace"
+        assert 1.3 < time.monotonic() - begun < 120.0, "a film is played at its own pace"
         assert session.states["following"] > 0 and 2 <= session.counts["frames"] <= 35
         assert not session.counts["malformed"] + session.counts["repeated"] + session.counts["late"]
         angle = np.arccos(np.clip((np.einsum("jab,jab->j", poses[-1], pose_of(figure)) - 1) / 2, -1, 1))
@@ -98,7 +98,7 @@ def test_a_camera_that_is_unplugged_stops_the_robot_and_ends_the_session(cv2: An
         run_session(session)
     assert poses and session.last is not None and session.last.state == "ended"
     assert not session.last.velocity_N.any(), "it has braked"
-    until = time.monotonic() + 60.0  # a look at a picture that has begun is ended, however busy the machine is
+    until = time.monotonic() + 180.0  # a look at a picture that has begun is ended, however busy the machine is
     while [thread for thread in threading.enumerate() if thread.name.startswith("camera")]:
         assert time.monotonic() < until, "a thread goes on"
         time.sleep(0.01)
@@ -178,7 +178,7 @@ def test_a_film_that_shows_one_picture_for_long_ends_at_once(tmp_path: Path, fig
     path = write_video(tmp_path / "film.mkv", [figure, figure, figure], [0, 40, 60_000])
     session, _ = followed(CameraSource(film=path, model="lite"))
     run_session(session, 0.5)
-    until = time.monotonic() + 60.0  # a look at a picture that has begun is ended, however busy the machine is
+    until = time.monotonic() + 180.0  # a look at a picture that has begun is ended, however busy the machine is
     while [thread for thread in threading.enumerate() if thread.name.startswith("camera")]:
         assert time.monotonic() < until, "a thread goes on"
         time.sleep(0.01)

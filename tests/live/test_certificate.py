@@ -59,7 +59,7 @@ def who_trusts(path: Path) -> ssl.SSLContext:
 def test_a_client_that_was_told_of_it_checks_it_and_comes_in(server: Server, ours: ServerCertificate) -> None:
     port = server.endpoint.port
     for host in ("127.0.0.1", "localhost"):
-        page = http.client.HTTPSConnection(host, port, timeout=30, context=who_trusts(ours.path))
+        page = http.client.HTTPSConnection(host, port, timeout=120, context=who_trusts(ours.path))
         page.connect()
         assert page.sock.version() in ("TLSv1.2", "TLSv1.3")  # pyright: ignore[reportAttributeAccessIssue]
         page.request("GET", "/")
@@ -77,10 +77,10 @@ def test_a_client_that_was_told_of_it_checks_it_and_comes_in(server: Server, our
 
 
 def test_who_was_not_told_refuses_it(server: Server) -> None:
-    stranger = http.client.HTTPSConnection("127.0.0.1", server.endpoint.port, timeout=30)
+    stranger = http.client.HTTPSConnection("127.0.0.1", server.endpoint.port, timeout=120)
     with pytest.raises(ssl.SSLCertVerificationError, match="self-signed"):
         stranger.request("GET", "/")
-    plain = http.client.HTTPConnection("127.0.0.1", server.endpoint.port, timeout=30)
+    plain = http.client.HTTPConnection("127.0.0.1", server.endpoint.port, timeout=120)
     with pytest.raises((http.client.HTTPException, OSError)):
         plain.request("GET", "/")
         plain.getresponse()

@@ -37,7 +37,7 @@ def held(browser: Browser, open_server: Server) -> Iterator[Callable[[bool], Non
     inbox = Inbox(10.0)
 
     def wait(wanted: bool) -> None:
-        end = time.monotonic() + 60
+        end = time.monotonic() + 180
         while True:
             open_server.take(inbox, time.monotonic())
             if inbox.held == wanted == (browser.ask("document.getElementById('hold').ariaPressed") == "true"):

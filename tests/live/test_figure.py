@@ -42,7 +42,7 @@ def server(nao: Robot) -> Iterator[Server]:
 
 
 def ask(server: Server, path: str) -> tuple[int, bytes]:
-    connection = http.client.HTTPConnection("127.0.0.1", server.endpoint.port, timeout=30)
+    connection = http.client.HTTPConnection("127.0.0.1", server.endpoint.port, timeout=120)
     connection.request("GET", path)
     answer = connection.getresponse()
     return answer.status, answer.read()

@@ -72,7 +72,7 @@ class Listener:
         self.server, self.inbox = server, Inbox(10.0)
 
     def until(self, true: Any, what: str) -> None:
-        end = time.monotonic() + 20
+        end = time.monotonic() + 120
         while not true():
             assert time.monotonic() < end, what
             self.server.take(self.inbox, time.monotonic())

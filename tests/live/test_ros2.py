@@ -20,7 +20,7 @@ from mrhubo.live.sinks.ros2 import Ros2Sink
 from mrhubo.live.sinks.trajectory import trajectory
 from tests.live.robots import AT_ONCE, NAMES, make_robot
 
-_PATIENCE_S = 20.0
+_PATIENCE_S = 120.0
 
 
 class _Kind:

@@ -23,7 +23,7 @@ from mrhubo.live.server import PageSource, Server
 from mrhubo.live.visitors import Visitors, find_file
 from tests.live.messages import beat, message
 
-_PATIENCE = 30.0
+_PATIENCE = 120.0
 """Seconds: on a busy machine a thread may wait for its turn."""
 
 

@@ -62,7 +62,7 @@ def deaths(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "        work_on(open_study(Path(sys.argv[1]) / str(drawn), None, 's', 'random', 0), die, 2)\n"
         "    assert os.waitpid(child, 0)[1] == 9, 'killed'"
     )
-    subprocess.run([sys.executable, "-c", code, str(folder)], timeout=120, check=True)
+    subprocess.run([sys.executable, "-c", code, str(folder)], timeout=300, check=True)
     return folder
 
 

@@ -86,7 +86,7 @@ def test_a_picture_that_does_not_come_is_left_out(asked: list[Any], monkeypatch:
     begun = time.monotonic()
     with pytest.raises(UserError, match="camera 0: is gone"):
         next(pictures)
-    assert 0.4 < time.monotonic() - begun < 5.0
+    assert 0.4 < time.monotonic() - begun < 60.0
 
 
 @pytest.mark.parametrize("device", ["", "film.mp4", "http://127.0.0.1/", "/dev/video999", "-1", "1234", "0 1", "²"])

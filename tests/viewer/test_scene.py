@@ -126,7 +126,7 @@ def test_the_page_is_served_until_it_is_enough(stage: Stage, capsys: pytest.Capt
     enough = threading.Event()
 
     def look(address: str) -> None:
-        with urllib.request.urlopen(address, timeout=10) as page:
+        with urllib.request.urlopen(address, timeout=60) as page:
             found.extend([address, page.read(200_000).decode()])
         enough.set()
 

@@ -761,7 +761,7 @@ def test_a_small_file_cannot_ask_for_much(motion: Motion, tmp_path: Path) -> Non
             read(parts.glb(), tmp_path)
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()
-        assert peak < 400e6 and time.monotonic() - begun < 10
+        assert peak < 400e6 and time.monotonic() - begun < 60
 
 
 def test_the_beginning_tells_gltf(motion: Motion, tmp_path: Path) -> None:
