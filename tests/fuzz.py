@@ -54,7 +54,7 @@ from tests.motion.readers import (
     test_soma_and_points,
     test_trc_file,
 )
-from tests.motion.readers.markers import test_convert, test_segments
+from tests.motion.readers.markers import test_convert, test_recording, test_segments
 from tests.robot_motion.motions import standing
 from tests.robot_motion.test_broken_files import robot_motion_read_or_refused
 
@@ -259,7 +259,9 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "trc": ("damaged.trc", lambda path: path.write_text(test_trc_file.trc(test_trc_file.places()))),
     "points.pkl": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"keypoints3d": _points()}))),
     "take": ("damaged.json", _take),
-    "matlab": ("damaged.mat", lambda path: savemat(path, {"fps": 30.0, **_bones()}, do_compression=True)),
+    "matlab": ("damaged.mat", lambda path: savemat(path, {"fps": 30.0, **_bones()})),
+    "matlab, packed": ("damaged.mat", lambda path: savemat(path, {"fps": 30.0, **_bones()}, do_compression=True)),
+    "recording": ("damaged.mat", lambda path: savemat(path, {"take": test_recording.recording()})),
     "points by joint": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"fps": 30.0, **_bones()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},

@@ -24,6 +24,7 @@ from mrhubo.motion.readers.keypoint_files import checked
 from mrhubo.motion.readers.keypoint_json import points_of_frames
 from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.layouts import find_layout
+from mrhubo.motion.readers.markers.recording import read_recording
 from mrhubo.motion.readers.motionstreamer import read_streamed
 from mrhubo.motion.readers.nymeria import read_nymeria
 from mrhubo.motion.readers.options import ReadOptions
@@ -73,7 +74,8 @@ def read_estimated(path: Path, options: ReadOptions) -> Motion:
         return find_rate(path, (tree, *(child for _, child in first_entries(tree))), options, notes)
 
     found = (
-        read_rows(tree, options)
+        read_recording(tree, options)
+        or read_rows(tree, options)
         or read_bare_poses(tree, options)
         or read_features(tree, options)
         or read_interhuman(tree, options)

@@ -45,7 +45,7 @@ def points_beside_names(tree: Tree, options: ReadOptions) -> Keypoints | None:
         if shape is None or len(shape) != 3 or shape[1:] != (len(names), 3) or not shape[0]:
             continue
         point_TK3 = child.array()
-        if point_TK3.dtype.kind in "fiu" and _is_body(point_TK3.astype(np.float64), names):
+        if point_TK3.dtype.kind in "fiu" and is_body(point_TK3.astype(np.float64), names):
             found = Keypoints(point_TK3.astype(np.float64), names, where=f"'{key}'", notes=options.of_one())
             told = rate_in(tree, found.notes)
             found.rate = None if told is None else told[1]
@@ -107,7 +107,7 @@ def _in_node(node: Tree) -> Keypoints | None:
     if len(frames) != 1 or not by_names(list(places)).keys() >= set(NEEDED):
         return None
     point_TK3 = np.stack(list(places.values()), axis=1)
-    if not are_called and not _is_body(point_TK3, list(places)):
+    if not are_called and not is_body(point_TK3, list(places)):
         return None
     sure_TK = np.stack([sure[name] for name in places], axis=1) if sure.keys() == places.keys() else None
     where = f"'{node.where}'" if node.where else "the arrays"
@@ -132,8 +132,8 @@ def _place(node: Tree) -> tuple[np.ndarray | None, bool]:
 
 
 @np.errstate(all="ignore")
-def _is_body(point_TK3: np.ndarray, names: Sequence[str]) -> bool:
-    """Whether upper arms and thighs keep their lengths, and those are a body's."""
+def is_body(point_TK3: np.ndarray, names: Sequence[str]) -> bool:
+    """Whether upper arms and thighs of points (T, K, 3) keep their lengths, and those are a body's."""
     points = {name: point_TK3[:, place] for name, place in by_names(names).items()}
     lengths = []
     for start, end in (("shoulder", "elbow"), ("hip", "knee")):

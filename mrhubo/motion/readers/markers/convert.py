@@ -71,7 +71,7 @@ def read_c3d(path: Path, options: ReadOptions) -> Motion:
 
 
 def motion_of_labelled(path: Path, found: Keypoints, kind: str, options: ReadOptions) -> Motion:
-    """The motion of one of those whose points a file has by labels, `LASI` or `Ann:LASI`.
+    """The motion of one of those whose points a file has by labels, `LASI`, `Ann:LASI` or `Ann_LASI`.
 
     Args:
         path: the file.
@@ -86,14 +86,16 @@ def motion_of_labelled(path: Path, found: Keypoints, kind: str, options: ReadOpt
     labels = found.names or []
     people = _people(labels)
     if len(people) > 1:
-        seen = {name: int(np.isfinite(found.point_TK3[:, at]).all(-1).any(-1).sum()) for name, at in people.items()}
-        columns = people[
+        seen = {
+            name: int(np.isfinite(found.point_TK3[:, list(at)]).all(-1).any(-1).sum()) for name, at in people.items()
+        }
+        of_one = people[
             choose(path, [Person(name, count) for name, count in seen.items()], options, found.notes).person
         ]
     else:
-        columns = next(iter(people.values()), list(range(len(labels))))
+        of_one = next(iter(people.values()), dict(enumerate(labels)))
         found.notes.extend(options.of_one() if options.person not in people else [])
-    one = replace(found, point_TK3=found.point_TK3[:, columns], names=[labels[column] for column in columns])
+    one = replace(found, point_TK3=found.point_TK3[:, list(of_one)], names=list(of_one.values()))
     if has_body(one.names or []):
         return motion_of_markers(path, one, kind, options)
     if _are_joints(one.names or []):
@@ -153,13 +155,22 @@ def _levelled(motion: Motion) -> Motion:
     return motion.changed(local_TJ33=turn_feet(arrays.local_TJ33, (left_3, right_3)))
 
 
-def _people(labels: Sequence[str]) -> dict[str, list[int]]:
-    """The columns of those who have the points of a body, by what is before a colon."""
-    heads: dict[str, list[int]] = {}
-    for column, label in enumerate(labels):
-        heads.setdefault(label.rpartition(":")[0], []).append(column)
-    named = {head: [labels[column] for column in columns] for head, columns in heads.items()}
-    return {head: columns for head, columns in heads.items() if has_body(named[head]) or _are_joints(named[head])}
+def _people(labels: Sequence[str]) -> dict[str, dict[int, str]]:
+    """Of those who have the points of a body, the columns and their labels, by what is before a colon, or else before
+    the first low line, as skeletons of Qualisys Track Manager have it.
+    """
+    for parts in ([label.rpartition(":") for label in labels], [label.partition("_") for label in labels]):
+        heads: dict[str, dict[int, str]] = {}
+        for column, (head, mark, rest) in enumerate(parts):
+            heads.setdefault(head if mark else "", {})[column] = rest if mark else head or rest
+        people = {head: named for head, named in heads.items() if _is_somebody(list(named.values()))}
+        if people:
+            return people
+    return {}
+
+
+def _is_somebody(labels: Sequence[str]) -> bool:
+    return has_body(labels) or _are_joints(labels)
 
 
 def _are_joints(names: Sequence[str]) -> bool:
