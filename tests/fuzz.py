@@ -52,6 +52,7 @@ from tests.motion.readers import (
     test_pose_folders,
     test_sam3d_folders,
     test_soma_and_points,
+    test_table_header,
     test_trc_file,
 )
 from tests.motion.readers.markers import test_convert, test_recording, test_segments
@@ -262,6 +263,8 @@ READERS: dict[str, tuple[str, Callable[[Path], object]]] = {
     "matlab": ("damaged.mat", lambda path: savemat(path, {"fps": 30.0, **_bones()})),
     "matlab, packed": ("damaged.mat", lambda path: savemat(path, {"fps": 30.0, **_bones()}, do_compression=True)),
     "recording": ("damaged.mat", lambda path: savemat(path, {"take": test_recording.recording()})),
+    "table under two lines": ("damaged.csv", lambda path: path.write_text(test_table_header.spreadsheet())),
+    "table of triples": ("damaged.csv", lambda path: path.write_text(test_table_header.total_capture())),
     "points by joint": ("damaged.pkl", lambda path: path.write_bytes(pickle.dumps({"fps": 30.0, **_bones()}))),
     "points.npy": ("damaged.npy", lambda path: np.save(path, _points())),
     **{name: (f"damaged{w.ending}", _estimator(name)) for name, w in estimator_files.WRITERS.items()},

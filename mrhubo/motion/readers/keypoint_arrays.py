@@ -31,7 +31,8 @@ POINT_KEYS = (
 between words do not matter: `keypoints3D` is `keypoints_3d`, `poseWorldLandmarks` is `pose_world_landmarks`.
 """
 _PLAIN = {key.replace("_", ""): place for place, key in enumerate(POINT_KEYS)}
-NAME_KEYS = ("names", "joint_names", "keypoint_names", "landmark_names", "keypoints_names")
+NAME_KEYS = ("names", "joint_names", "keypoint_names", "landmark_names", "keypoints_names", "jointNames",
+             "keypointNames", "landmarkNames")  # fmt: skip
 CONFIDENCE_KEYS = ("confidence", "confidences", "conf", "scores", "visibility", "keypoint_scores", "presence")
 LIFT = "lift them to three dimensions first, for instance with MMPose or MotionBERT"
 """What to do with points in a picture."""
@@ -89,10 +90,15 @@ def points_of_rows(tree: Tree, shape: tuple[int, ...]) -> np.ndarray | None:
     for numbers in (3, 4):
         if shape[1] % numbers == 0:
             point_TKX = array.reshape(len(array), -1, numbers)
-            fits = fitting_sets(known_points(point_TKX[:: 1 + len(array) // _SAMPLED, :, :3].astype(np.float64)))
-            if fits and fits[0][0] < NONSENSE:
+            if is_known_body(point_TKX[..., :3]):
                 return point_TKX
     return None
+
+
+def is_known_body(point_TK3: np.ndarray) -> bool:
+    """Whether points make a body in the order of a set that is known."""
+    fits = fitting_sets(known_points(point_TK3[:: 1 + len(point_TK3) // _SAMPLED].astype(np.float64)))
+    return bool(fits) and fits[0][0] < NONSENSE
 
 
 def may_be_points(shape: tuple[int, ...]) -> bool:

@@ -21,6 +21,7 @@ from mrhubo.motion.readers.keypoint_arrays import (
     NAME_KEYS,
     Keypoints,
     in_array,
+    is_known_body,
     may_be_points,
     of_one_person,
     point_key,
@@ -38,6 +39,8 @@ _KINECT_RATE = 30.0
 """Frames a second of NTU RGB+D's motions."""
 _DEEPEST, _MOST_CLIPS, _FEWEST_POINTS = 2, 10_000, 12
 """Dictionaries in dictionaries of clips, clips in them, and points of a body."""
+_FEW = 20
+"""Entries of a dictionary beside one array, at most."""
 
 
 def in_npz(tree: Tree, options: ReadOptions) -> Keypoints:
@@ -67,7 +70,7 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
         if rows is not None:
             return in_array(path, tree, options, rows)
         return in_array(path, tree, options) if shape is not None and may_be_points(shape) else None
-    found = _samples(tree, options) or points_by_joint(tree, options)
+    found = _samples(tree, options) or points_by_joint(tree, options) or _alone(tree, options)
     if found is not None:
         return found
     if point_key(tree.keys) is not None and not tree[_key(tree)].is_mapping:
@@ -163,6 +166,26 @@ def _time_first(array: np.ndarray, points: int) -> np.ndarray:
         if array.shape[:2] == (3, points):
             return array.transpose(2, 1, 0)
     return array
+
+
+def _alone(tree: Tree, options: ReadOptions) -> Keypoints | None:
+    """The points of the only array in a dictionary, whatever it is called, if its last axis is that of the frames and
+    they make a body in the order of a set that is known: UTD-MHAD's `d_skel` (20, 3, T)
+    (https://personal.utdallas.edu/~kehtar/UTD-MHAD.html); None of any other.
+    """
+    shapes = {} if len(tree) > _FEW else {name: node.shape() for name, node in tree.items() if not node.is_mapping}
+    arrays = [name for name, shape in shapes.items() if shape is not None and len(shape) > 1]
+    shape = shapes[arrays[0]] if len(arrays) == 1 else None
+    if shape is None or len(shape) != 3 or 3 not in shape[:2] or shape[2] in (0, 3, 4):
+        return None
+    array = tree[arrays[0]].array()
+    if array.dtype.kind not in "fiu":
+        return None
+    point_TK3 = _time_first(array, shape[0] if shape[1] == 3 else shape[1]).astype(np.float64)
+    if not is_known_body(point_TK3):
+        return None
+    told = rate_in(tree, notes := options.of_one())
+    return Keypoints(point_TK3, rate=None if told is None else told[1], where=f"'{arrays[0]}'", notes=notes)
 
 
 def _key(node: Tree) -> str:

@@ -46,6 +46,8 @@ each part of that way is: of people in motions 0.97 and 0.13."""
 _SPINE_OVER_THIGH, _HIPS_OVER_THIGH, _HIPS_HIGH = (0.5, 1.6), (0.2, 0.8), 1.2
 """How long that way is, how far apart hips are, and how far the pelvis is at most from between them as a share of that;
 of the bodies of SMPL's family 1.0 to 1.1, 0.33 to 0.44, and 0.83."""
+_PELVIS_AWAY = 0.6
+"""How far the pelvis is from between the hips at most, as a share of the way from there to between the shoulders."""
 _FLABBY = 0.2
 """Half of the frames are farther from a bone's usual length than this share of it: of points drawn by chance."""
 
@@ -67,7 +69,7 @@ def misfit(points: Mapping[str, np.ndarray]) -> float:
     chance has it.
     """
     found: list[float] = []
-    if points.keys() >= {"spine1", "head"} and (_is_short(points) or _has_no_trunk(points)):
+    if points.keys() >= {"spine1", "head"} and (_is_short(points) or _has_no_trunk(points)) or _is_headlong(points):
         return np.inf
     with np.errstate(all="ignore"):
         way = {
@@ -120,6 +122,17 @@ def _has_no_trunk(points: Mapping[str, np.ndarray]) -> bool:
         and _HIPS_OVER_THIGH[0] < hips < _HIPS_OVER_THIGH[1]
         and high < _HIPS_HIGH
     )
+
+
+def _is_headlong(points: Mapping[str, np.ndarray]) -> bool:
+    """Whether the pelvis is far from the hips in the middle of the frames; in an order from the head it may be that."""
+    if not points.keys() >= {"pelvis", *(f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip"))}:
+        return False
+    hips_F3, shoulders_F3 = ((points[f"left_{joint}"] + points[f"right_{joint}"]) / 2 for joint in ("hip", "shoulder"))
+    with np.errstate(all="ignore"):
+        share_F = np.linalg.norm(points["pelvis"] - hips_F3, axis=-1) / np.linalg.norm(shoulders_F3 - hips_F3, axis=-1)
+    seen_F = share_F[np.isfinite(share_F)]
+    return bool(len(seen_F)) and float(np.median(seen_F)) > _PELVIS_AWAY
 
 
 def _is_short(points: Mapping[str, np.ndarray]) -> bool:

@@ -17,7 +17,7 @@ from mrhubo.motion.readers.keypoint_arrays import LIFT, point_key
 
 _PEOPLE = ("instances", "people", "bodies", "body_list", "object_list", "persons", "skeletons", "actors")
 _SURE = ("visibility", "confidence", "score", "presence")
-_MORE_POINTS = ("jointdata", "bones", "bodyparts", "transforms", "body")
+_MORE_POINTS = ("jointdata", "bones", "bodyparts", "transforms", "body", "jointmodeltransforms", "jointtransforms")
 """What frames call points beside what arrays of them are called."""
 _PLACES = (
     "position",
@@ -29,6 +29,10 @@ _PLACES = (
     "coordinates",
     "coords",
     "xyz",
+    "transform",
+    "modeltransform",
+    "worldtransform",
+    "matrix",
 )
 """What a point that has more than a place, as a bone's rotation, calls that."""
 _NAMES = ("name", "jointname", "joint", "bonename", "bone", "label", "part", "keypoint", "landmark")
@@ -71,6 +75,8 @@ def people_of(frame: Any) -> list[Any] | None:
     first = frame[0] if isinstance(frame, list) and frame else None
     if isinstance(first, dict):
         return frame if points_key(first) is not None else None
+    if isinstance(first, list) and _translation(first) is not first:
+        return None
     return frame if isinstance(first, list) and first and isinstance(first[0], dict | list) else None
 
 
@@ -97,6 +103,7 @@ def row_of(path: Path, where: str, number: int, frame: Any) -> Row:
             point = _listed(point)
         if isinstance(point, list) and len(point) == 2 and all(isinstance(part, list) for part in point):
             point = point[0]  # a bone's place, and its rotation
+        point = _translation(point)
         if point is None:
             point = [None, None, None]
         if not isinstance(point, list) or len(point) not in (3, 4):
@@ -139,6 +146,22 @@ def _listed(point: dict[str, Any]) -> Any:
         place = [by_axis.get(axis) for axis in "xyz"]
     sure = next((plain[key] for key in _SURE if key in plain), None)
     return [*place, sure] if sure is not None and isinstance(place, list) and len(place) == 3 else place
+
+
+def _translation(point: Any) -> Any:
+    """The place of a joint's axes in a matrix of 16 numbers, or 4 times 4, of rows or, as ARKit's, of columns; anything
+    else as it is.
+    """
+    if not isinstance(point, list) or len(point) not in (4, 16):
+        return point
+    flat = point
+    if len(point) == 4:
+        if not all(isinstance(part, list) and len(part) == 4 for part in point):
+            return point
+        flat = [number for part in point for number in part]
+    if not all(type(number) in (int, float) for number in flat) or flat[15] != 1:
+        return point
+    return flat[12:15] if not any(flat[3:15:4]) else flat[3:15:4] if not any(flat[12:15]) else point
 
 
 def _plain(key: Any) -> str:

@@ -9,7 +9,8 @@ Kinect https://learn.microsoft.com/azure/kinect-dk/body-joints; MPI-INF-3DHP htt
 CMU Panoptic http://domedb.perception.cs.cmu.edu; SPIN's https://github.com/nkolot/SPIN/blob/master/constants.py, of
 which 4D-Humans keeps the first 44; the 45, 73, 127 and 144 of the package smplx https://github.com/vchoutas/smplx, of
 SMPL, SMPL-H and SMPL-X; Stereolabs' ZED with 34 and 38 https://www.stereolabs.com/docs/body-tracking; Kinect 1
-https://learn.microsoft.com/previous-versions/windows/kinect-1.8/jj131025(v=ieb.10); NVIDIA Maxine
+https://learn.microsoft.com/previous-versions/windows/kinect-1.8/jj131025(v=ieb.10), and as UTD-MHAD has it
+https://personal.utdallas.edu/~kehtar/UTD-MHAD.html; NVIDIA Maxine
 https://docs.nvidia.com/maxine/ar/latest/Appendix/B3DBodyPoseKeypointFormat.html; LSP
 http://sam.johnson.io/research/lsp.html; KIT-ML as HumanML3D's authors have it
 https://github.com/EricGuo5513/HumanML3D; MPII http://human-pose.mpi-inf.mpg.de. FreeMoCap and others put MediaPipe's
@@ -95,6 +96,7 @@ SETS: dict[str, tuple[str, ...]] = {
         "left_knee right_knee left_ankle right_ankle left_toe right_toe - - left_heel right_heel - - left_index "
         "right_index - - left_pinky right_pinky",
         "Kinect 1": f"pelvis spine2 - - {_KINECT}",
+        "Kinect 1 from the head": f"head neck spine2 pelvis {_KINECT}",
         "Kinect 2": f"pelvis spine2 - - {_KINECT} - - - - -",
         "NVIDIA Maxine": "pelvis left_hip right_hip spine2 left_knee right_knee neck left_ankle right_ankle left_toe "
         "right_toe - - left_heel right_heel nose left_eye right_eye left_ear right_ear left_shoulder right_shoulder "

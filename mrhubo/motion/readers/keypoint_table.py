@@ -3,8 +3,8 @@
 FreeMoCap's `mediapipe_body_3d_xyz.csv` has `left_shoulder_x`, `left_shoulder_y`, `left_shoulder_z` and so on, in
 millimetres (https://github.com/freemocap/freemocap); who writes landmarks of MediaPipe into a table by hand calls them
 so, or `x_left_shoulder`, or `x1`, `y1`, `z1`, `v1`, or `0_x`, or `landmark_0_x`. Columns stand between commas,
-semicolons (numbers then may have decimal commas) or tabs. Tables with a line a point are read by
-`mrhubo.motion.readers.point_table`.
+semicolons (numbers then may have decimal commas) or tabs. Headers of several lines are made one by
+`mrhubo.motion.readers.table_header`; tables with a line a point are read by `mrhubo.motion.readers.point_table`.
 
 Legend: T frames, K keypoints.
 """
@@ -31,8 +31,10 @@ from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import NEEDED, by_names
 from mrhubo.motion.readers.rate import rate_of_even, rate_of_seconds
 from mrhubo.motion.readers.sightings import check_size, placed
+from mrhubo.motion.readers.table_header import separator_of, with_one_header
 
-_KINDS = {"x": 0, "y": 1, "z": 2, "v": 3, "visibility": 3, "confidence": 3, "conf": 3, "score": 3, "presence": 3}
+_KINDS = {"x": 0, "y": 1, "z": 2, "v": 3, "visibility": 3, "confidence": 3, "conf": 3, "score": 3, "presence": 3,
+          "likelihood": 3}  # fmt: skip
 """What stands behind, or before, the name of a point: an axis, or how sure it is."""
 _LAST = re.compile(r"(.+?)[ _.:\-\[(]*(?<![a-z])(" + "|".join(_KINDS) + r")[\])]?(?: *[\[(].*)?", re.IGNORECASE)
 _FIRST = re.compile(
@@ -52,6 +54,8 @@ NOTHING = ("", "nan", "none", "null", "na")
 _FEWEST = 5
 """Points that a table has at least."""
 _MAX_BYTES, _MAX_COLUMNS = 2**28, 10_000
+_BEGIN = 8
+"""Lines by which a table is known."""
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,7 @@ class _Header:
 
 def is_table(content: Content) -> bool:
     """Whether a text begins with a header of points in space."""
-    return content.text is not None and _read_header(_lines(content.text)[0]) is not None
+    return content.text is not None and _read_header(_lines(content.text, _BEGIN)[0]) is not None
 
 
 def read_table(path: Path, options: ReadOptions) -> Motion:
@@ -109,7 +113,7 @@ def read_table(path: Path, options: ReadOptions) -> Motion:
 
 def split_header(line: str) -> tuple[str, list[str]]:
     """What stands between the columns of a table, and their names; none where the line is no header."""
-    separator = max("\t;,", key=line.count)
+    separator = separator_of(line)
     try:
         return separator, next(csv.reader([line], delimiter=separator), [])
     except csv.Error:
@@ -164,8 +168,8 @@ def numbers_of(
     return np.array(found).reshape(len(rows), len(columns))
 
 
-def _lines(text: str) -> list[str]:
-    return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+def _lines(text: str, most: int | None = None) -> Sequence[str]:
+    return with_one_header(text.replace("\r\n", "\n").replace("\r", "\n").split("\n")[:most])
 
 
 def _read_header(line: str) -> _Header | None:

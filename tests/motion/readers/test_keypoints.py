@@ -451,6 +451,53 @@ def test_matlab(axes: str, points: dict[str, np.ndarray], pose: torch.Tensor, tm
     assert found.frame_rate == 50 and len(found) == FRAMES and bone_error(found, pose) < 5
 
 
+@pytest.mark.parametrize("frames_last", [False, True])
+def test_an_array_alone_with_the_frames_last(
+    frames_last: bool, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    """As UTD-MHAD has it; and what fits no body is none."""
+    path, array = tmp_path / "take.mat", array_of(points, SETS["Kinect 1 from the head"])
+    savemat(path, {"d_skel": array.transpose((1, 2, 0) if frames_last else (2, 1, 0))})
+    found = mrhubo.read_motion(path, RATE)
+    assert "'d_skel', 20 points as Kinect 1 from the head has them" in found.source and bone_error(found, pose) < 0.2
+    savemat(path, {"d_skel": np.random.default_rng(0).normal(size=(20, 3, FRAMES))})
+    with pytest.raises(mrhubo.motion.NoMotion, match="no human motion that is known here"):
+        mrhubo.read_motion(path, RATE)
+
+
+@pytest.mark.parametrize("rows", [True, False])
+@pytest.mark.parametrize("form", ["flat", "nested", "a key", "a list"])
+def test_places_in_matrices(
+    form: str, rows: bool, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
+) -> None:
+    """Of rows, or of columns, as iPhones' ARKit has them, by its names."""
+    parts = {"shoulder": "arm", "elbow": "forearm", "wrist": "hand", "hip": "upLeg", "knee": "leg", "ankle": "foot"}
+    names = {f"{side}_{ours}": f"{side}_{theirs}_joint" for side in SIDES for ours, theirs in parts.items()}
+    names |= {"pelvis": "hips_joint", "neck": "neck_1_joint", "head": "head_joint"}
+    turn_33 = np.array([[0.0, -1, 0], [0.8, 0, 0.6], [-0.6, 0, 0.8]])
+
+    def matrix(name: str, frame: int) -> Any:
+        matrix_44 = np.eye(4)
+        matrix_44[:3, :3], matrix_44[:3, 3] = turn_33, points[name][frame]
+        matrix_44 = matrix_44 if rows else matrix_44.T
+        told = matrix_44.tolist() if form == "nested" else matrix_44.ravel().tolist()
+        return {"name": names[name], "transform": told} if form == "a list" else told
+
+    frames = []
+    for frame in range(FRAMES):
+        joints = {names[name]: matrix(name, frame) for name in names}
+        frames.append(
+            {"timestamp": frame / 50, "jointModelTransforms" if form == "a key" else "joints": [*joints.values()]}
+            if form in ("a key", "a list")
+            else {"timestamp": frame / 50, "joints": joints}
+        )
+    path = tmp_path / "take.json"
+    path.write_text(json.dumps({"jointNames": list(names.values()), "frames": frames}))
+    found = mrhubo.read_motion(path)
+    assert found.frame_rate == pytest.approx(50) and bone_error(found, pose) < 5
+    assert found.root_position_T3 is not None
+
+
 @pytest.mark.parametrize("rotation", ["random", "zero", "still"])
 def test_rotations_by_joint_are_no_places(rotation: str, tmp_path: Path) -> None:
     random, still = np.random.default_rng(0), np.ones((FRAMES, 1))
