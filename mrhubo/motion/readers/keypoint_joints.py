@@ -24,6 +24,8 @@ from mrhubo.motion.readers.rate import rate_in
 
 _PLACES = ("position", "positions", "pos", "global_position", "global_positions", "world_position", "world_positions",
            "translation", "translations", "location", "locations", "xyz")  # fmt: skip
+_VALUES = ("frames", "values", "data", "samples")
+"""What files may call places too, or rotations."""
 _MOST = 1_000
 """Entries of a dictionary of joints."""
 _STEADY, _ALIKE = 0.2, 0.2
@@ -117,13 +119,14 @@ def _in_node(node: Tree) -> Keypoints | None:
 def _place(node: Tree) -> tuple[np.ndarray | None, bool]:
     """Where a joint is (T, 3), and whether it is called that; None where a node tells no places."""
     called = node.get(*_PLACES) if node.is_mapping else None
-    if called is None and node.is_mapping:
+    chosen = node.get(*_VALUES) if called is None and node.is_mapping else called
+    if chosen is None and node.is_mapping:
         axes = [node.find_array(axis) for axis in "xyz"]
         shapes = {None if axis is None else axis.shape for axis in axes}
         if len(shapes) > 1 or None in shapes or len(next(iter(shapes)) or ()) != 1:
             return None, False
         return np.stack([axis for axis in axes if axis is not None], axis=-1).astype(np.float64), True
-    chosen = node if called is None else called
+    chosen = node if chosen is None else chosen
     shape = None if chosen.is_mapping else chosen.shape()
     if shape is None or len(shape) != 2 or shape[1] != 3 or not shape[0]:
         return None, False

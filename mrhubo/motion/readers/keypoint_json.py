@@ -145,10 +145,18 @@ def _rate_of_frames(numbers: Sequence[int], frames: Sequence[Any]) -> float | No
     if list(numbers) != list(range(len(numbers))):
         return None
     for key in (*TIME_KEYS, "t"):
-        times = [frame.get(key) if isinstance(frame, dict) else None for frame in frames]
+        times = [_under(frame, key) for frame in frames]
         if all(type(time) in (int, float) for time in times):
             return rate_of_even(np.array(times))
     return None
+
+
+def _under(frame: Any, key: str) -> Any:
+    """What a frame has under a key, or the scene that is all that it has."""
+    if not isinstance(frame, dict):
+        return None
+    inner = next(iter(frame.values())) if len(frame) == 1 else None
+    return inner.get(key) if key not in frame and isinstance(inner, dict) else frame.get(key)
 
 
 def _frames(path: Path, where: str, value: Any) -> list[tuple[int, Any]]:

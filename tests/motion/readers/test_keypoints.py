@@ -407,7 +407,9 @@ def test_names_beside_an_array_tell_whatever_they_are_called(
     assert found.frame_rate == 50 and f"'{keys[0]}'" in found.source and bone_error(found, pose) < 5
 
 
-@pytest.mark.parametrize("form", ["places", "places and rotations", "named", "of a scene", "joints in a list"])
+@pytest.mark.parametrize(
+    "form", ["places", "places and rotations", "named", "of a scene", "joints in a list", "frames of joints"]
+)
 def test_frames_of_bones_in_other_containers(
     form: str, points: dict[str, np.ndarray], pose: torch.Tensor, tmp_path: Path
 ) -> None:
@@ -421,9 +423,11 @@ def test_frames_of_bones_in_other_containers(
         value = {"frames": [{"joints": place_K3, "root": still} for place_K3 in array], "names": list(ours.values())}
     elif form == "of a scene":
         people = [[{"name": "Ann", "body": {n: {"position": x} for n, x in frame.items()}}] for frame in value]
-        value = [{"scene": {"actors": here, "timestamp": 0.1}} for here in people]
+        value = [{"scene": {"actors": here, "timestamp": 2 + place / 25}} for place, here in enumerate(people)]
     elif form == "joints in a list":
         value = {"joints": [{"name": n, "positions": array[:, i]} for i, n in enumerate(ours.values())]}
+    elif form == "frames of joints":
+        value = {"joints": [{"joint": n, "frames": array[:, i].tolist()} for i, n in enumerate(ours.values())]}
     path.write_bytes(pickle.dumps(value))
     found = mrhubo.read_motion(path, RATE)
     assert len(found) == FRAMES and bone_error(found, pose) < 5
@@ -431,6 +435,7 @@ def test_frames_of_bones_in_other_containers(
         path = tmp_path / "take.json"
         path.write_text(json.dumps(value, default=lambda array: array.tolist()))
         assert mrhubo.read_motion(path, RATE).checksum == found.checksum
+        assert mrhubo.read_motion(path).frame_rate == pytest.approx(25)
         with pytest.raises(UserError, match="Ben"):
             mrhubo.read_motion(tmp_path / "take.pkl", ReadOptions(rate=30, person="Ben"))
 
