@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -27,7 +28,7 @@ from mrhubo.motion.readers.point_names import NEEDED, by_names
 from mrhubo.motion.readers.tracks import Person, choose
 
 _SKELETONS, _TRAJECTORIES, _RATE = "Skeletons", "Trajectories", "FrameRate"
-_MOST = 1_000
+_MOST = 100
 """Recordings in a file, and skeletons in a recording."""
 
 
@@ -83,9 +84,9 @@ def _is_recording(keys: Sequence[str]) -> bool:
 def _entries(tree: Tree) -> Iterator[Tree]:
     """The file's dictionary, those in it, and those in lists in it."""
     yield tree
-    for _, child in list(tree.items())[:_MOST]:
+    for _, child in islice(tree.items(), _MOST):
         yield child
-        yield from list(child)[:_MOST]
+        yield from islice(child, _MOST)
 
 
 def _rate(node: Tree) -> float | None:
@@ -98,7 +99,7 @@ def _rate(node: Tree) -> float | None:
 def _skeletons(node: Tree) -> Iterator[_Skeleton]:
     """Those with the segments of a body."""
     home = node.get(_SKELETONS)
-    for number, one in enumerate([] if home is None else [home, *list(home)[:_MOST]]):
+    for number, one in enumerate([] if home is None else [home, *islice(home, _MOST)]):
         labels, places = one.get("SegmentLabels"), one.get("PositionData")
         if labels is None or places is None:
             continue
