@@ -104,6 +104,7 @@ class Session:
                 f"held up: {pauses} times for longer than stop_time, in which the robot stopped; the machine is busy,"
                 " or a sink waits"
             )
+        more += [silences] if (silences := self.pilot.silences.told()) else []
         return "\n".join([f"sent: {sent or 'nothing'}\nreceived: {came or 'nothing'}", *more])
 
     @classmethod

@@ -21,6 +21,7 @@ from mrhubo.live.messages import Landmarks, Nobody
 from mrhubo.live.output import Output
 from mrhubo.live.robot import LiveRobot
 from mrhubo.live.roots import Jumped
+from mrhubo.live.silences import Silences
 from mrhubo.live.walk import Walk
 
 
@@ -50,6 +51,7 @@ class Pilot:
         """When the last moment was [s]."""
         self.pauses = 0
         """How often a period took longer than `stop_time`, so that the robot had stopped by itself."""
+        self.silences = Silences(config, frames_are_deadman)
         self._body = Body(has_legs=robot.standing is not None)
         self._handedness = Handedness()
         self._answer_N, self._confidence_X = robot.home_N, np.zeros(len(robot.branch_names))
@@ -78,6 +80,8 @@ class Pilot:
             if self.legs is not None:
                 self.legs.settle()
             self._going_since = None
+        if now - self._ticked > self.config.heartbeat_timeout:
+            self.silences.skip()
         self._ticked = now
         frame = self.inbox.take_frame()
         if frame is not None and not self._ended:
@@ -150,6 +154,7 @@ class Pilot:
         inbox = self.inbox
         last = inbox.frame_at if self._frames_are_deadman else inbox.heartbeat_at
         held = self._frames_are_deadman or inbox.held
+        self.silences.hear(last, held and not self._ended)
         return held and not self._ended and now - last <= self.config.heartbeat_timeout
 
     def _ramp(self, passed: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import signal
 import socket
 from pathlib import Path
@@ -182,6 +183,34 @@ def test_a_signal_stops_the_robot_and_then_interrupts(clock: Clock, replay: Repl
     finally:
         signal.signal(number, before)
     assert not is_still(sink.outputs[99]) and is_still(sink.outputs[-1]) and len(sink.outputs) < 115
+
+
+@pytest.mark.parametrize("of_frames", [True, False])
+@pytest.mark.parametrize("apart", [0.05, 0.25])
+def test_what_comes_too_seldom_is_told(clock: Clock, apart: float, of_frames: bool) -> None:
+    class Slow(NamedSource):
+        """Somebody who is seen, and a button that is held, now and then; and released at last."""
+
+        has_heartbeat, sent = not of_frames, 0
+
+        def read(self, inbox: Inbox, now: float) -> bool:
+            if (now - 100.0) / apart > self.sent:
+                self.sent += 1
+                inbox.offer(message(2 * self.sent, time=now), "a", now)
+                if not of_frames:
+                    inbox.offer(beat(2 * self.sent + 1, held=now < 103.0, time=now), "a", now)
+            return now < 104.0
+
+    session = loop.run(random_robot(0), [Slow()], [Kept()], LiveConfig(ramp_time=0.0))
+    told = session.summary().split("\n")[-1]
+    if apart < LiveConfig().heartbeat_timeout:
+        assert "silence" not in session.summary()
+        return
+    count = 16 if of_frames else 11  # none while it is not held
+    assert re.match(rf"stopped for silence: {count} times, as a \w+ came 0.25 s after the last, .* is 0.1 s; ", told), (
+        told
+    )
+    assert ("a button" in told) == of_frames and "heartbeat_timeout=0.18 stop_time=0.3" in told
 
 
 def test_it_ends_after_some_time(clock: Clock, replay: ReplaySource) -> None:
