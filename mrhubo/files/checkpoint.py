@@ -117,12 +117,13 @@ def to_tensor(value: Any, storages: dict[str, bytes]) -> Tensor:
     """The tensor that a pickled one stands for, float32; raises what `numbers_of` does."""
     import torch
 
-    return torch.from_numpy(numbers_of(value, storages))
+    with np.errstate(over="ignore"):
+        return torch.from_numpy(numbers_of(value, storages).astype(np.float32))
 
 
 def numbers_of(value: Any, storages: dict[str, bytes]) -> np.ndarray:
-    """The numbers of the tensor that a pickled one stands for, float32. PyTorch, which takes a second to import, is not
-    needed for that.
+    """The numbers of the tensor that a pickled one stands for, of its type: times since 1970 are not exact in less.
+    PyTorch, which takes a second to import, is not needed for that.
 
     Raises:
         UserError: it stands for something else, or reaches beyond its storage.
@@ -150,8 +151,7 @@ def numbers_of(value: Any, storages: dict[str, bytes]) -> np.ndarray:
             raise UserError(f"a tensor has shape {shape} and stride {stride}")
         if last >= len(numbers) or math.prod(shape) > len(numbers):
             raise UserError(f"a tensor of shape {shape} reaches beyond its {len(numbers)} numbers")
-        with np.errstate(over="ignore"):
-            numbers = numbers[offset : last + 1].astype(np.float32)
+        numbers = numbers[offset : last + 1]
         strides = [step * numbers.itemsize for step in stride]
         return np.lib.stride_tricks.as_strided(numbers, shape, strides).copy()
     except UserError:

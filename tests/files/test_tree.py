@@ -95,6 +95,17 @@ def test_what_torch_and_numpy_save(tmp_path: Path) -> None:
     check(found["all"])
 
 
+@pytest.mark.parametrize("dump", [torch.save, lambda value, path: path.write_bytes(pickle.dumps(value))])
+def test_tensors_keep_their_types(dump: Any, tmp_path: Path) -> None:
+    """Times since 1970, in seconds and nanoseconds, are not exact in less."""
+    times = {"s": torch.arange(5, dtype=torch.float64) / 30 + 1.7e9, "ns": torch.arange(5) * 33_333_333 + 1700 * 10**15}
+    dump(times | {"half": torch.ones(2).half(), "yes": torch.tensor([True, False])}, tmp_path / "a.pt")
+    found = read_tree(tmp_path / "a.pt")
+    for name, tensor in times.items():
+        np.testing.assert_array_equal(found[name].array(), tensor.numpy())
+    assert found["half"].array().tolist() == [1, 1] and found["yes"].array().tolist() == [1, 0]
+
+
 @pytest.mark.parametrize("value", [10**400, [10**400], [[0.5], [-(10**400)]]])
 def test_whole_numbers_that_no_float_is_as_large_as(tmp_path: Path, value: Any) -> None:
     (tmp_path / "a.pkl").write_bytes(pickle.dumps({"pose": value}))
