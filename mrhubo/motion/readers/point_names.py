@@ -28,6 +28,8 @@ _CENTRAL = {
     "head": "head", "head_top": "headtop tophead top headtopend headend",
 }  # fmt: skip
 _SPINE = ("spine1", "spine2", "spine3")
+_HIGH = 0.48
+"""How high `spine2` is on the way from the pelvis to the neck."""
 _OF_NO_POINT = ("mixamorig", "bip", "def", "position", "pos", "loc", "location", "world", "joint", "jnt", "marker")
 """Words that say of which program a name is, or that it is a place."""
 NEEDED = [f"{side}_{joint}" for side in SIDES for joint in ("shoulder", "hip")]
@@ -55,22 +57,31 @@ def by_names(names: Sequence[str]) -> dict[str, int]:
         told = _told(name)
         if told is not None:
             found.setdefault(told, place)
-    plain = [name.rpartition(":")[2].strip().lower() for name in names]
-    if found.get("spine2") == next((place for place, name in enumerate(plain) if name == "spine"), -1) and (
-        "spine1" in found
-    ):
-        _raise_spine(found, plain)
+    _count_spine(found, names)
     for side in SIDES:
         _bones_to_points(found, side)
     return found
 
 
-def _raise_spine(found: dict[str, int], plain: list[str]) -> None:
-    """Spines of animations, which are counted from a first one without a number."""
-    chain = [plain.index("spine"), found["spine1"], *(plain.index(name) for name in ("spine2",) if name in plain)]
+def _count_spine(found: dict[str, int], names: Sequence[str]) -> None:
+    """Spines of animations, whose joints are counted, from a first one that may have no number; of more than three, the
+    one that is as high as ours alone.
+    """
+    chain: dict[int, int] = {}
+    for place, name in enumerate(names):
+        words = _words(name.rpartition(":")[2])
+        if "spine" in words and all(word == "spine" or (word.isdecimal() and len(word) < 4) for word in words):
+            chain.setdefault(next((int(word) for word in words if word != "spine"), -1), place)
+    places = [chain[number] for number in sorted(chain)]
+    ours = any(_told(names[place]) in _SPINE[::2] for place in places) and -1 not in chain
+    if len(places) < 2 or (ours and len(places) <= len(_SPINE)):
+        return
     for name in _SPINE:
         found.pop(name, None)
-    found.update(zip(_SPINE, chain, strict=False))
+    if len(places) <= len(_SPINE):
+        found.update(zip(_SPINE, places, strict=False))
+    else:
+        found["spine2"] = places[round(_HIGH * (len(places) + 1)) - 1]
 
 
 def _bones_to_points(found: dict[str, int], side: str) -> None:
@@ -100,8 +111,7 @@ def _told(name: str) -> str | None:
         return plain
     if plain.replace("_", "") in _SPINE:
         return plain.replace("_", "")
-    words = [word.lower() for word in _WORD.findall(bare)]
-    words = [word for word in words if word not in _OF_NO_POINT] or words
+    words = _words(bare)
     side = next((our for our, theirs in (("left", _LEFT), ("right", _RIGHT)) if set(words) & set(theirs)), None)
     rest = "".join(word for word in words if word not in (*_LEFT, *_RIGHT) and not word.isdigit())
     if side is None:
@@ -111,3 +121,9 @@ def _told(name: str) -> str | None:
         side, rest = {"l": "left", "r": "right"}[rest[0]], rest[1:]
     part = next((our for our, theirs in _PARTS.items() if rest in theirs.split()), None)
     return None if part is None else f"{side}_{part}"
+
+
+def _words(bare: str) -> list[str]:
+    """The words of a name in small letters, without those that say nothing of a point."""
+    words = [word.lower() for word in _WORD.findall(bare)]
+    return [word for word in words if word not in _OF_NO_POINT] or words

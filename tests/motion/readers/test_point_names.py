@@ -60,5 +60,22 @@ def test_spines_are_counted_from_the_first() -> None:
     assert by_names(["Pelvis", "Spine", "Neck"]) == {"pelvis": 0, "spine2": 1, "neck": 2}
 
 
+@pytest.mark.parametrize(
+    ("names", "wanted"),
+    [
+        (["spine_01", "spine_02", "spine_03"], {"spine1": 0, "spine2": 1, "spine3": 2}),
+        (["Spine1_Loc", "Spine2_Loc"], {"spine1": 0, "spine2": 1}),
+        (["spine2", "spine3"], {"spine2": 0, "spine3": 1}),
+        ([f"spine_0{number}" for number in (3, 1, 2, 5, 4)], {"spine2": 0}),
+        ([f"spine_{number}_joint" for number in range(1, 8)], {"spine2": 3}),
+        (["Spine", "Spine1", "Spine2", "Spine3"], {"spine2": 1}),
+        (["Spine", "Spine99999999999999999999"], {"spine2": 0}),
+    ],
+)
+def test_of_many_joints_of_a_spine_the_middle_is_ours(names: list[str], wanted: dict[str, int]) -> None:
+    """Unreal's and ARKit's; the lowest of five leans as the loin, and not as the chest."""
+    assert by_names(names) == wanted
+
+
 def test_a_bone_alone_is_no_point() -> None:
     assert our_name("LeftArm") is None and our_name("LeftLeg") is None and our_name("LeftShin") == "left_knee"
