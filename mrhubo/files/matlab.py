@@ -66,8 +66,6 @@ def read_matlab(path: Path) -> dict[str, Any]:
             raise _Damaged("its header does not tell the order of its bytes")
         return _Reader(order).variables(content)
     except (_Damaged, zlib.error, ValueError, OverflowError) as error:
-        if isinstance(error, UserError):
-            raise
         raise UserError(f"is a MATLAB file that is damaged: {error}") from error
 
 
@@ -200,7 +198,7 @@ class _Reader:
         return [text[row :: sizes[0]].rstrip() for row in range(sizes[0])]
 
     def _cells(self, elements: _Elements, sizes: Sequence[int], depth: int) -> Any:
-        return self._nested([self._value(elements, depth) for _ in range(_count(sizes, elements.left))], sizes)
+        return _nested([self._value(elements, depth) for _ in range(_places(sizes, elements.left))], sizes)
 
     def _structures(self, elements: _Elements, sizes: Sequence[int], depth: int) -> Any:
         width, names = elements.numbers(), elements.next()[1]
@@ -210,8 +208,8 @@ class _Reader:
         fields = [_until_zero(names[begin : begin + step]) for begin in range(0, len(names), step)]
         if not fields:
             return {}
-        made = [{name: self._value(elements, depth) for name in fields} for _ in range(_count(sizes, elements.left))]
-        return self._nested(made, sizes)
+        made = [{name: self._value(elements, depth) for name in fields} for _ in range(_places(sizes, elements.left))]
+        return _nested(made, sizes)
 
     def _value(self, elements: _Elements, depth: int) -> Any:
         kind, content = elements.next()
@@ -219,18 +217,9 @@ class _Reader:
             raise _Damaged(f"it has an element {kind} where a variable is expected")
         return self._matrix(content, depth)[1]
 
-    def _nested(self, values: list[Any], sizes: Sequence[int]) -> Any:
-        """Lists in lists; what is alone by itself."""
-        if len(values) == 1:
-            return values[0]
-        table = np.empty(len(values), dtype=object)
-        for number, value in enumerate(values):
-            table[number] = value
-        return _of_matrix(table, sizes).tolist()
 
-
-def _count(sizes: Sequence[int], left: int) -> int:
-    """Of cells or structures, each of which takes 8 bytes at least."""
+def _places(sizes: Sequence[int], left: int) -> int:
+    """How many cells or structures there are, each of which takes 8 bytes at least."""
     count = math.prod(sizes)
     if count > left // 8:
         raise _Damaged("it ends early")
@@ -241,6 +230,16 @@ def _of_matrix(values: np.ndarray, sizes: Sequence[int]) -> np.ndarray:
     """Of these sizes, column after column; MATLAB knows no array of fewer than two axes."""
     shaped = values.reshape(sizes, order="F")
     return shaped.reshape([size for size in sizes if size != 1]) if len(sizes) == 2 else shaped
+
+
+def _nested(values: list[Any], sizes: Sequence[int]) -> Any:
+    """Lists in lists; what is alone by itself."""
+    if len(values) == 1:
+        return values[0]
+    table = np.empty(len(values), dtype=object)
+    for number, value in enumerate(values):
+        table[number] = value
+    return _of_matrix(table, sizes).tolist()
 
 
 def _until_zero(content: memoryview) -> str:

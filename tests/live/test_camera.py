@@ -75,6 +75,14 @@ def followed(source: CameraSource) -> tuple[Session, list[np.ndarray]]:
     return Session.of(make_robot(answer), [source], [], CONFIG), poses
 
 
+def no_thread_goes_on() -> None:
+    """Of a source that is closed; a look at a picture that has begun is ended, however busy the machine is."""
+    until = time.monotonic() + 180.0
+    while [thread for thread in threading.enumerate() if thread.name.startswith("camera")]:
+        assert time.monotonic() < until, "a thread goes on"
+        time.sleep(0.01)
+
+
 def test_a_film_is_followed_as_if_a_camera_saw_it(film: Path, figure: np.ndarray) -> None:
     needs_models()
     source = CameraSource(film=film, model="lite")
@@ -98,10 +106,7 @@ def test_a_camera_that_is_unplugged_stops_the_robot_and_ends_the_session(cv2: An
         run_session(session)
     assert poses and session.last is not None and session.last.state == "ended"
     assert not session.last.velocity_N.any(), "it has braked"
-    until = time.monotonic() + 180.0  # a look at a picture that has begun is ended, however busy the machine is
-    while [thread for thread in threading.enumerate() if thread.name.startswith("camera")]:
-        assert time.monotonic() < until, "a thread goes on"
-        time.sleep(0.01)
+    no_thread_goes_on()
 
 
 def test_the_newest_picture_counts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -178,10 +183,7 @@ def test_a_film_that_shows_one_picture_for_long_ends_at_once(tmp_path: Path, fig
     path = write_video(tmp_path / "film.mkv", [figure, figure, figure], [0, 40, 60_000])
     session, _ = followed(CameraSource(film=path, model="lite"))
     run_session(session, 0.5)
-    until = time.monotonic() + 180.0  # a look at a picture that has begun is ended, however busy the machine is
-    while [thread for thread in threading.enumerate() if thread.name.startswith("camera")]:
-        assert time.monotonic() < until, "a thread goes on"
-        time.sleep(0.01)
+    no_thread_goes_on()
 
 
 def test_a_damaged_film_ends_the_session_with_a_sentence(film: Path, tmp_path: Path) -> None:

@@ -30,7 +30,7 @@ from mrhubo.motion.readers.keypoint_arrays import (
 )
 from mrhubo.motion.readers.keypoint_joints import names_beside, points_beside_names, points_by_joint
 from mrhubo.motion.readers.options import ReadOptions
-from mrhubo.motion.readers.rate import rate_in, rate_of_all
+from mrhubo.motion.readers.rate import frames_a_second, rate_of_all
 from mrhubo.motion.readers.tracks import Person, choose
 
 _SAMPLES, _LENGTHS = "motion", "lengths"
@@ -90,8 +90,8 @@ def points_in(tree: Tree, options: ReadOptions) -> Keypoints | None:
         others = set(people) - {track.person for track in tracks}
         notes.append(f"left out, as there are no points of frames in them: {shortened(listed(others), 200)}")
     found = _named_in(people[choose(path, tracks, options, notes).person], ReadOptions())
-    if found.rate is None and (told := rate_in(tree, found.notes)) is not None:
-        found.rate = told[1]
+    if found.rate is None:
+        found.rate = frames_a_second(tree, found.notes)
     found.notes += notes
     return found
 
@@ -153,8 +153,7 @@ def _in_node(path: Path, node: Tree, options: ReadOptions) -> Keypoints:
         ):
             confidence = confidence.take(number, axis)
         found.confidence_TK = np.asarray(confidence, dtype=np.float64)
-    told = rate_in(node, found.notes)
-    found.rate = None if told is None else told[1]
+    found.rate = frames_a_second(node, found.notes)
     return found
 
 
@@ -184,8 +183,8 @@ def _alone(tree: Tree, options: ReadOptions) -> Keypoints | None:
     point_TK3 = _time_first(array, shape[0] if shape[1] == 3 else shape[1]).astype(np.float64)
     if not is_known_body(point_TK3):
         return None
-    told = rate_in(tree, notes := options.of_one())
-    return Keypoints(point_TK3, rate=None if told is None else told[1], where=f"'{arrays[0]}'", notes=notes)
+    rate = frames_a_second(tree, notes := options.of_one())
+    return Keypoints(point_TK3, rate=rate, where=f"'{arrays[0]}'", notes=notes)
 
 
 def _key(node: Tree) -> str:

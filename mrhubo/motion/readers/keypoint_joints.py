@@ -20,7 +20,7 @@ from mrhubo.files.tree import Tree
 from mrhubo.motion.readers.keypoint_arrays import CONFIDENCE_KEYS, Keypoints
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import NEEDED, by_names
-from mrhubo.motion.readers.rate import rate_in
+from mrhubo.motion.readers.rate import frames_a_second
 
 _PLACES = ("position", "positions", "pos", "global_position", "global_positions", "world_position", "world_positions",
            "translation", "translations", "location", "locations", "xyz")  # fmt: skip
@@ -49,8 +49,7 @@ def points_beside_names(tree: Tree, options: ReadOptions) -> Keypoints | None:
         point_TK3 = child.array()
         if point_TK3.dtype.kind in "fiu" and is_body(point_TK3.astype(np.float64), names):
             found = Keypoints(point_TK3.astype(np.float64), names, where=f"'{key}'", notes=options.of_one())
-            told = rate_in(tree, found.notes)
-            found.rate = None if told is None else told[1]
+            found.rate = frames_a_second(tree, found.notes)
             return found
     return None
 
@@ -77,8 +76,7 @@ def points_by_joint(tree: Tree, options: ReadOptions) -> Keypoints | None:
         node = _under_names(node)
         if 0 < len(node.keys) <= _MOST and (found := _in_node(node)) is not None:
             found.notes = options.of_one()
-            told = rate_in(tree, found.notes) or rate_in(node, found.notes)
-            found.rate = None if told is None else told[1]
+            found.rate = frames_a_second(tree, found.notes) or frames_a_second(node, found.notes)
             return found
     return None
 

@@ -36,7 +36,7 @@ from mrhubo.motion.readers.keypoint_joints import points_beside_names, points_by
 from mrhubo.motion.readers.keypoint_rows import NOTHING, Row, people_of, points_key, row_of
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import NEEDED, by_names
-from mrhubo.motion.readers.rate import TIME_KEYS, rate_in, rate_of_even
+from mrhubo.motion.readers.rate import TIME_KEYS, frames_a_second, rate_of_even
 from mrhubo.motion.readers.sightings import Sighting, check_size, frames_of_one, person_called
 
 _FRAMES = ("instance_info", "frames", "data")
@@ -91,8 +91,8 @@ def points_of_json(path: Path, value: Any, options: ReadOptions) -> Keypoints:
     meta = whole.get("meta_info") if isinstance(whole, dict) else None
     if found.names is None:
         found.names = _names_of(names, meta, found.point_TK3.shape[1])
-    told = rate_in(tree, found.notes)
-    found.rate = _rate_of_frames(numbers, frames) if told is None else told[1]
+    rate = frames_a_second(tree, found.notes)
+    found.rate = _rate_of_frames(numbers, frames) if rate is None else rate
     return found
 
 

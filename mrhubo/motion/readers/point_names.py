@@ -73,6 +73,7 @@ def _count_spine(found: dict[str, int], names: Sequence[str]) -> None:
         if "spine" in words and all(word == "spine" or (word.isdecimal() and len(word) < 4) for word in words):
             chain.setdefault(next((int(word) for word in words if word != "spine"), -1), place)
     places = [chain[number] for number in sorted(chain)]
+    # ours are told by their numbers, whichever are there: `spine2` and `spine3` alone are no first and second
     ours = any(_told(names[place]) in _SPINE[::2] for place in places) and -1 not in chain
     if len(places) < 2 or (ours and len(places) <= len(_SPINE)):
         return

@@ -90,6 +90,12 @@ def rate_in(node: Tree, notes: list[str]) -> tuple[str, float] | None:
     return None
 
 
+def frames_a_second(node: Tree, notes: list[str]) -> float | None:
+    """What `rate_in` finds, whatever the key."""
+    told = rate_in(node, notes)
+    return None if told is None else told[1]
+
+
 def rate_of_times(node: Tree) -> float | None:
     """Frames per second of evenly spaced times, in seconds, milli-, micro- or nanoseconds; None of any other."""
     try:

@@ -17,9 +17,9 @@ _FEWEST, _DEEPEST = 5, 6
 """Points of a table, and lines of a header at most."""
 
 
-def separator_of(line: str) -> str:
-    """What stands between the columns of a table, by its first line."""
-    return max("\t;,", key=line.count)
+def separator_of(text: str) -> str:
+    """What stands between the columns of a table, by some of its lines."""
+    return max("\t;,", key=text.count)
 
 
 def with_one_header(lines: Sequence[str]) -> Sequence[str]:
@@ -54,7 +54,7 @@ def _of_triples(lines: Sequence[str]) -> list[str] | None:
 def _of_rows(lines: Sequence[str]) -> list[str] | None:
     if not lines:
         return None
-    separator = max((separator_of(line) for line in lines[:_DEEPEST]), key="\n".join(lines[:_DEEPEST]).count)
+    separator = separator_of("\n".join(lines[:_DEEPEST]))
     rows = [_cells(line, separator) for line in lines[: _DEEPEST + 1]]
     for place, row in enumerate(rows[1:_DEEPEST], start=1):
         axes = {column: found for column, cell in enumerate(row) if (found := _AXIS.fullmatch(cell)) is not None}

@@ -133,6 +133,14 @@ def choose(path: Path, tracks: Sequence[Chosen], options: ReadOptions, notes: li
     return chosen
 
 
+def choose_or_only(path: Path, tracks: Sequence[Chosen], options: ReadOptions, notes: list[str]) -> Chosen:
+    """As `choose`; but whoever is there alone is taken whatever name is asked for, and a note says so."""
+    if len(tracks) != 1 or options.person == tracks[0].person:
+        return choose(path, tracks, options, notes)
+    notes += options.of_one()
+    return tracks[0]
+
+
 def motion_of(path: Path, arrays: SmplArrays, kind: Kind, frame_rate: float, notes: list[str]) -> Motion:
     """A person's motion, from the first frame in which they are seen to the last; between, where they are not, it goes
     from one frame to the next with a confidence of 0.

@@ -11,29 +11,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import mrhubo
-from mrhubo.body.joints import JOINT_NAMES, SIDES
+from mrhubo.body.joints import JOINT_NAMES
 from mrhubo.motion import NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.table_header import with_one_header
-from tests.motion.readers.markers.bodies import moving_body
+from tests.motion.readers.markers.bodies import BONES, moving_body
 from tests.motion.readers.markers.test_convert import limbs_off
-
-_NAMES = {
-    "Hips": "pelvis", "Spine": "spine1", "Spine1": "spine2", "Spine2": "spine3", "Neck": "neck", "Head": "head",
-} | {
-    f"{side.capitalize()}{theirs}": f"{side}_{ours}"
-    for side in SIDES
-    for theirs, ours in (
-        ("Shoulder", "collar"), ("Arm", "shoulder"), ("ForeArm", "elbow"), ("Hand", "wrist"), ("UpLeg", "hip"), ("Leg", "knee"),
-        ("Foot", "ankle"),
-    )
-}  # fmt: skip
 
 
 def rows() -> list[list[list[float]]]:
     """Places of joints, frame by frame."""
     place_TJ3 = moving_body("boxing")[0]
-    return [[place_TJ3[t, JOINT_NAMES.index(ours)].tolist() for ours in _NAMES.values()] for t in range(len(place_TJ3))]
+    return [[place_TJ3[t, JOINT_NAMES.index(ours)].tolist() for ours in BONES.values()] for t in range(len(place_TJ3))]
 
 
 def _words(numbers: Sequence[float], sign: str) -> str:
@@ -42,14 +31,14 @@ def _words(numbers: Sequence[float], sign: str) -> str:
 
 def total_capture() -> str:
     lines = ["\t".join(_words([x / 0.0254 for x in place], " ") for place in row) + "\t" for row in rows()]
-    return "\n".join(["\t".join(_NAMES) + "\t", *lines, ""])
+    return "\n".join(["\t".join(BONES) + "\t", *lines, ""])
 
 
 def deeplabcut() -> str:
     head = [
-        "scorer" + ",DLC_3D" * (3 * len(_NAMES)),
-        "bodyparts," + ",".join(name for name in _NAMES for _ in "xyz"),
-        "coords" + ",x,y,z" * len(_NAMES),
+        "scorer" + ",DLC_3D" * (3 * len(BONES)),
+        "bodyparts," + ",".join(name for name in BONES for _ in "xyz"),
+        "coords" + ",x,y,z" * len(BONES),
     ]
     return "\n".join([*head, *(f"{t},{_words(sum(row, []), ',')}" for t, row in enumerate(rows()))])
 
@@ -57,10 +46,10 @@ def deeplabcut() -> str:
 def spreadsheet(sign: str = ",", units: bool = True) -> str:
     """A name over the first of its axes, times, units, and a title."""
     head = [
-        "Take 3" + sign * (3 * len(_NAMES) + 1),
-        sign.join(["Frame", "Time", *(name + 2 * sign for name in _NAMES)]),
-        sign.join(["", "", *("X", "Y", "Z") * len(_NAMES)]),
-        *([sign.join(["", "s", *("m",) * (3 * len(_NAMES))])] if units else []),
+        "Take 3" + sign * (3 * len(BONES) + 1),
+        sign.join(["Frame", "Time", *(name + 2 * sign for name in BONES)]),
+        sign.join(["", "", *("X", "Y", "Z") * len(BONES)]),
+        *([sign.join(["", "s", *("m",) * (3 * len(BONES))])] if units else []),
     ]
     lines = [f"{t}{sign}{t / 50}{sign}{_words(sum(row, []), sign)}" for t, row in enumerate(rows())]
     return "\n".join([*head, *lines])
@@ -98,6 +87,6 @@ def test_other_lines_stay(text: str) -> None:
 
 
 def test_a_plain_header_stays() -> None:
-    header = ",".join(f"{name}_{axis}" for name in _NAMES for axis in "xyz")
+    header = ",".join(f"{name}_{axis}" for name in BONES for axis in "xyz")
     lines = [header, *(_words(np.ravel(row), ",") for row in rows())]
     assert with_one_header(lines) is lines

@@ -28,7 +28,7 @@ from mrhubo.motion.readers.markers.segments import has_segments, motion_of_segme
 from mrhubo.motion.readers.names import motion_name
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import NEEDED, by_names
-from mrhubo.motion.readers.tracks import Person, check_span, choose
+from mrhubo.motion.readers.tracks import Person, check_span, choose_or_only
 
 _STANDS_FOR = {"shoulder": "acromion", "hip": "front_pelvis", "knee": "lateral_knee", "ankle": "lateral_ankle"}
 """Markers near joints, by which up, left and the unit are told."""
@@ -85,16 +85,12 @@ def motion_of_labelled(path: Path, found: Keypoints, kind: str, options: ReadOpt
     """
     labels = found.names or []
     people = _people(labels)
-    if len(people) > 1:
-        seen = {
-            name: int(np.isfinite(found.point_TK3[:, list(at)]).all(-1).any(-1).sum()) for name, at in people.items()
-        }
-        of_one = people[
-            choose(path, [Person(name, count) for name, count in seen.items()], options, found.notes).person
-        ]
+    if people:
+        seen = [Person(name, _seen(found.point_TK3[:, list(columns)])) for name, columns in people.items()]
+        of_one = people[choose_or_only(path, seen, options, found.notes).person]
     else:
-        of_one = next(iter(people.values()), dict(enumerate(labels)))
-        found.notes.extend(options.of_one() if options.person not in people else [])
+        of_one = dict(enumerate(labels))
+        found.notes.extend(options.of_one())
     one = replace(found, point_TK3=found.point_TK3[:, list(of_one)], names=list(of_one.values()))
     if has_body(one.names or []):
         return motion_of_markers(path, one, kind, options)
@@ -167,6 +163,11 @@ def _people(labels: Sequence[str]) -> dict[str, dict[int, str]]:
         if people:
             return people
     return {}
+
+
+def _seen(point_TK3: np.ndarray) -> int:
+    """In how many frames any of some points is seen."""
+    return int(np.isfinite(point_TK3).all(-1).any(-1).sum())
 
 
 def _is_somebody(labels: Sequence[str]) -> bool:

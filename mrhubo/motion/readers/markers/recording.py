@@ -15,7 +15,6 @@ from itertools import islice
 
 import numpy as np
 
-from mrhubo.errors import UserError
 from mrhubo.files.tree import Tree
 from mrhubo.motion.motion import Motion
 from mrhubo.motion.readers.content import NoMotion
@@ -25,7 +24,8 @@ from mrhubo.motion.readers.keypoints import motion_of_points
 from mrhubo.motion.readers.markers.convert import motion_of_labelled
 from mrhubo.motion.readers.options import ReadOptions
 from mrhubo.motion.readers.point_names import NEEDED, by_names
-from mrhubo.motion.readers.tracks import Person, choose
+from mrhubo.motion.readers.rate import number_told
+from mrhubo.motion.readers.tracks import Person, choose_or_only
 
 _SKELETONS, _TRAJECTORIES, _RATE = "Skeletons", "Trajectories", "FrameRate"
 _MOST = 100
@@ -51,14 +51,10 @@ def read_recording(tree: Tree, options: ReadOptions) -> Motion | None:
     node, notes = recordings[0], list[str]()
     if len(recordings) > 1:
         notes.append(f"there are {len(recordings)} recordings in the file; the first is taken, '{node.where}'")
-    rate = _rate(node)
+    rate = number_told(node[_RATE])
     skeletons = list(_skeletons(node))
     if skeletons:
-        if len(skeletons) > 1 or options.person == skeletons[0].person:
-            chosen = choose(tree.path, skeletons, options, notes)
-        else:
-            chosen = skeletons[0]
-            notes += options.of_one()
+        chosen = choose_or_only(tree.path, skeletons, options, notes)
         if not is_body(chosen.place_TS3, chosen.names):
             raise NoMotion(
                 f"{tree.path}: '{chosen.person}' has limbs that do not keep their lengths, or are no person's; were its"
@@ -87,13 +83,6 @@ def _entries(tree: Tree) -> Iterator[Tree]:
     for _, child in islice(tree.items(), _MOST):
         yield child
         yield from islice(child, _MOST)
-
-
-def _rate(node: Tree) -> float | None:
-    try:
-        return node[_RATE].number()
-    except UserError:
-        return None
 
 
 def _skeletons(node: Tree) -> Iterator[_Skeleton]:

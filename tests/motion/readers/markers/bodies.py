@@ -8,10 +8,23 @@ from pathlib import Path
 import numpy as np
 
 import mrhubo
-from mrhubo.body.joints import OFFSETS_J3, PARENTS
+from mrhubo.body.joints import OFFSETS_J3, PARENTS, SIDES
 
 _MOTIONS = Path(__file__).resolve().parents[4] / "data/motions"
 _FRAMES = 60
+Z_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""From a world with y up, z forward, to one with z up, x forward."""
+BONES = {
+    "Hips": "pelvis", "Spine": "spine1", "Spine1": "spine2", "Spine2": "spine3", "Neck": "neck", "Head": "head",
+} | {
+    f"{side.capitalize()}{theirs}": f"{side}_{ours}"
+    for side in SIDES
+    for theirs, ours in (
+        ("Shoulder", "collar"), ("Arm", "shoulder"), ("ForeArm", "elbow"), ("Hand", "wrist"), ("UpLeg", "hip"),
+        ("Leg", "knee"), ("Foot", "ankle"),
+    )
+}  # fmt: skip
+"""Joints by the bones that begin there, as animations call them."""
 
 
 @functools.cache

@@ -18,14 +18,12 @@ from mrhubo.motion import Motion, NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from tests.motion.damage import Step, accidents, altered_words, damaged, read_or_refused
 from tests.motion.marker_writer import Manner, c3d, label_of, markers_on, qualisys, vicon
-from tests.motion.readers.markers.bodies import moving_body
+from tests.motion.readers.markers.bodies import Z_UP, moving_body
 from tests.motion.readers.test_trc_file import trc
-
-_Z_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 
 def marked(
-    markers: Mapping[str, np.ndarray] | None = None, unit: float = 1000.0, world_33: np.ndarray = _Z_UP
+    markers: Mapping[str, np.ndarray] | None = None, unit: float = 1000.0, world_33: np.ndarray = Z_UP
 ) -> tuple[np.ndarray, list[str]]:
     """Points (T, K, 3) of somebody who boxes, and their labels; in millimetres with z up, unless said otherwise."""
     markers = markers_on(*moving_body("boxing")) if markers is None else markers

@@ -15,35 +15,22 @@ from mrhubo.body.joints import JOINT_NAMES
 from mrhubo.motion import NoMotion
 from mrhubo.motion.readers.options import ReadOptions
 from tests.motion.marker_writer import c3d, qualisys
-from tests.motion.readers.markers.bodies import moving_body
+from tests.motion.readers.markers.bodies import BONES, Z_UP, moving_body
 from tests.motion.readers.markers.test_convert import limbs_off, marked
 from tests.motion.readers.markers.test_convert import read as read_file
-
-_Z_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-_SEGMENTS = {
-    "Hips": "pelvis", "Spine": "spine1", "Spine1": "spine2", "Spine2": "spine3", "Neck": "neck", "Head": "head",
-    **{
-        f"{side}{segment}": f"{side.lower()}_{joint}"
-        for side in ("Left", "Right")
-        for segment, joint in (
-            ("Shoulder", "collar"), ("Arm", "shoulder"), ("ForeArm", "elbow"), ("Hand", "wrist"), ("UpLeg", "hip"),
-            ("Leg", "knee"), ("Foot", "ankle"),
-        )
-    },
-}  # fmt: skip
 
 
 def skeleton(name: str = "Ann", unseen: slice = slice(0)) -> dict[str, Any]:
     """One that is solved, in millimetres with z up."""
-    place_TJ3 = 1000 * moving_body("boxing")[0] @ _Z_UP.T
-    places = np.stack([place_TJ3[:, JOINT_NAMES.index(joint)] for joint in _SEGMENTS.values()], axis=1)
+    place_TJ3 = 1000 * moving_body("boxing")[0] @ Z_UP.T
+    places = np.stack([place_TJ3[:, JOINT_NAMES.index(joint)] for joint in BONES.values()], axis=1)
     places[unseen] = np.nan
     return {
         "SkeletonName": name,
-        "NrOfSegments": len(_SEGMENTS),
-        "SegmentLabels": np.array([list(_SEGMENTS)], dtype=object),
+        "NrOfSegments": len(BONES),
+        "SegmentLabels": np.array([list(BONES)], dtype=object),
         "PositionData": places.transpose(2, 1, 0),
-        "RotationData": np.ones((4, len(_SEGMENTS), len(places))),
+        "RotationData": np.ones((4, len(BONES), len(places))),
     }
 
 

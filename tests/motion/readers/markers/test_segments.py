@@ -20,12 +20,11 @@ from mrhubo.motion.readers.markers.segments import joints_of
 from mrhubo.motion.readers.options import ReadOptions
 from tests.motion.damage import Step, accidents, damaged, read_or_refused
 from tests.motion.marker_writer import Manner, Segmented, c3d
-from tests.motion.readers.markers.bodies import moving_body
+from tests.motion.readers.markers.bodies import Z_UP, moving_body
 from tests.motion.readers.markers.test_convert import limbs_off, marked, read, world_turns
 
 _NO_POINTS = np.empty((60, 0, 3))
 _FLOATING = Manner(analog=0, rate=85.0)
-_Z_UP = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _LIMBS = {
     "thigh": ("hip", "knee"), "shank": ("knee", "ankle"), "uarm": ("shoulder", "elbow"), "larm": ("elbow", "wrist"),
 }  # fmt: skip
@@ -37,7 +36,7 @@ def axes(z_T3: np.ndarray, right_T3: np.ndarray) -> np.ndarray:
     return np.stack((x_T3, np.cross(z_T3, x_T3), z_T3), axis=-1)
 
 
-def theia(name: str = "boxing", unit: float = 1000.0, world_33: np.ndarray = _Z_UP) -> Segmented:
+def theia(name: str = "boxing", unit: float = 1000.0, world_33: np.ndarray = Z_UP) -> Segmented:
     """The segments of somebody, by the definitions of their axes: z up the limb, x the axis of elbow and knee, of a
     hand to the right where palms are turned forward.
     """
@@ -104,7 +103,7 @@ def test_frames_of_points_are_none_of_segments(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("unit", "world_33", "said"),
-    [(1000.0, _Z_UP, "millimetres, z up"), (1.0, np.eye(3), "metres, y up")],
+    [(1000.0, Z_UP, "millimetres, z up"), (1.0, np.eye(3), "metres, y up")],
 )
 def test_a_body_is_turned_as_its_segments(unit: float, world_33: np.ndarray, said: str, tmp_path: Path) -> None:
     motion = read(c3d(_NO_POINTS, [], _FLOATING, theia("boxing", unit, world_33)), tmp_path)
